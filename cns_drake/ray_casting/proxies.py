@@ -94,74 +94,81 @@ def make_proxies(members: Sequence[Member]) -> Proxies:
         elif not isinstance(surface, HalfSpaceSurface):
             curved.append((k, X_LG, surface))
     merged, owners = merge_triangles(flat)
-    corners, rows = _widen(merged)
     sides = _SIDES if len(curved) <= _MANY_SHAPES else _FEW_SIDES
     hulls, numbers = merge_triangles(
         [(k, m[1], circumscribe(m[2], sides)) for k, m in enumerate(curved)]
     )
-    records = np.zeros(len(rows) + len(numbers), _RECORD)
-    records["owner"][: len(rows)] = owners[rows]
-    records["owner"][len(rows) :] = np.array([m[0] for m in curved], np.int32)[
-        numbers
-    ]
-    records["shape"][: len(rows)] = -1
-    records["shape"][len(rows) :] = numbers
-    records["corners"][: len(rows)] = merged.p_GVset[merged.triangles[rows]]
+    # Memory takes longer than arithmetic, and what is not used is not taken.
+    most = 2 * len(merged.triangles) + len(numbers)
+    records = np.empty(most, _RECORD)
+    corners = np.empty((3 * most, 3), np.float32)
+    end = 0
+    for begin in range(0, len(merged.triangles), _BLOCK):
+        exact = merged.p_GVset[merged.triangles[begin : begin + _BLOCK]]
+        wide, rows = _widen(exact)
+        first, end = end, end + len(rows)
+        corners[3 * first : 3 * end] = wide.reshape(-1, 3)
+        block = records[first:end]
+        block["owner"] = owners[begin : begin + _BLOCK][rows]
+        block["shape"] = -1
+        block["corners"] = exact[rows]
+    first, end = end, end + len(numbers)
+    block = records[first:end]
+    block["owner"] = np.array([m[0] for m in curved], np.int32)[numbers]
+    block["shape"] = numbers
+    block["corners"] = 0.0
+    num_corners = 3 * first + len(hulls.p_GVset)
+    corners[3 * first : num_corners] = hulls.p_GVset
     return Proxies(
-        np.concatenate([corners, hulls.p_GVset.astype(np.float32)]),
+        corners[:num_corners],
         np.concatenate(
             [
-                np.arange(len(corners), dtype=np.uint32).reshape(-1, 3),
-                (hulls.triangles + len(corners)).astype(np.uint32),
+                np.arange(3 * first, dtype=np.uint32).reshape(-1, 3),
+                (hulls.triangles + 3 * first).astype(np.uint32),
             ]
         ),
-        records,
+        records[:end],
         np.array(
             [_shape_numbers(X, surface, sides) for _, X, surface in curved]
         ).reshape(-1, SHAPE_NUMBERS),
     )
 
 
-def _widen(surface: TriangleSurface) -> tuple[np.ndarray, np.ndarray]:
-    """Returns triangles that contain a margin around those of a surface.
+def _widen(corners: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Returns triangles that contain a margin around others.
+
+    Args:
+        corners: (N, 3, 3) corners of triangles [m].
 
     Returns:
-        (3 P, 3) float32 corners of P triangles [m]; and (P,) the triangle of
-        the surface that each contains.
+        (P, 3, 3) float32 corners of P triangles [m]; and (P,) the row of
+        `corners` that each contains, in rising order.
     """
-    parts = [np.zeros((0, 3, 3), np.float32)]
-    rows = [np.zeros(0, int)]
-    for begin in range(0, len(surface.triangles), _BLOCK):
-        corners = surface.p_GVset[surface.triangles[begin : begin + _BLOCK]]
-        a, b, c = (corners[:, k] for k in range(3))
-        opposite = [_length(c - b), _length(a - c), _length(b - a)]
-        around = opposite[0] + opposite[1] + opposite[2]
-        with np.errstate(divide="ignore", invalid="ignore"):
-            middle = (
-                opposite[0][:, None] * a
-                + opposite[1][:, None] * b
-                + opposite[2][:, None] * c
-            ) / around[:, None]
-            # Radius of the incircle, about which the triangle grows.
-            radius = _length(_cross(b - a, c - a)) / around
-            growth = np.maximum(_MARGIN / radius, _LEAST_SHARE)
-            reach = growth * np.maximum.reduce(opposite)
-            wide = corners + growth[:, None, None] * (corners - middle[:, None])
-        # No ray meets a triangle without area.
-        is_flat = ~(radius > 0.0)
-        wide[is_flat] = corners[is_flat]
-        parts.append(wide.astype(np.float32))
-        rows.append(begin + np.arange(len(wide)))
-        slender = np.flatnonzero(~is_flat & (reach > _FARTHEST))
-        if len(slender):
-            first, second = _rectangles(corners[slender])
-            parts[-1][slender] = first
-            parts.append(second.astype(np.float32))
-            rows.append(begin + slender)
-    triangles = np.concatenate(rows)
+    a, b, c = (corners[:, k] for k in range(3))
+    opposite = [_length(c - b), _length(a - c), _length(b - a)]
+    around = opposite[0] + opposite[1] + opposite[2]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        middle = (
+            opposite[0][:, None] * a
+            + opposite[1][:, None] * b
+            + opposite[2][:, None] * c
+        ) / around[:, None]
+        # Radius of the incircle, about which the triangle grows.
+        radius = _length(_cross(b - a, c - a)) / around
+        growth = np.maximum(_MARGIN / radius, _LEAST_SHARE)
+        reach = growth * np.maximum.reduce(opposite)
+        wide = corners + growth[:, None, None] * (corners - middle[:, None])
+    # No ray meets a triangle without area.
+    is_flat = ~(radius > 0.0)
+    wide[is_flat] = corners[is_flat]
+    wide = wide.astype(np.float32)
+    slender = np.flatnonzero(~is_flat & (reach > _FARTHEST))
+    wide[slender], second = _rectangles(corners[slender])
+    rows = np.concatenate([np.arange(len(wide)), slender])
     # The first of two shapes is hit where both are equally far.
-    order = np.argsort(triangles, kind="stable")
-    return np.concatenate(parts)[order].reshape(-1, 3), triangles[order]
+    order = np.argsort(rows, kind="stable")
+    wide = np.concatenate([wide, second.astype(np.float32)])
+    return wide[order], rows[order]
 
 
 def _rectangles(corners: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -12,7 +12,6 @@ from typing import cast
 from xml.etree import ElementTree
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from evaluation.base import (
     Element,
@@ -193,6 +192,9 @@ def _placed_meshes(root: Element) -> Iterator[tuple[Element, np.ndarray]]:
 
 def _own_place(node: Element) -> np.ndarray:
     """Returns the place (4, 4) of a node in its parent."""
+    # Slow to import, and most worlds have no such meshes.
+    from scipy.spatial.transform import Rotation
+
     X = np.eye(4)
     for one in node.all("*"):
         step = np.eye(4)

@@ -1,38 +1,6 @@
 """Notices changes of files."""
 
-from collections.abc import Callable
-import functools
 import os
-from pathlib import Path
-from typing import TypeVar
-
-# Larger files are read again each time, so that they do not stay in memory
-# [bytes].
-_SMALL = 1 << 18
-_Result = TypeVar("_Result")
-
-
-def once_a_file(
-    function: Callable[[Path], _Result],
-) -> Callable[[Path], _Result]:
-    """Makes a function read each small file once, unless the file changes.
-
-    The stages of a city share most of their files. All callers share the
-    results, which must therefore be read-only.
-    """
-
-    @functools.lru_cache(maxsize=4096)
-    def read_once(path: Path, stamp: tuple[int, ...]) -> _Result:
-        return function(path)
-
-    @functools.wraps(function)
-    def read(path: Path) -> _Result:
-        status = _status(path)
-        if status is None or status.st_size > _SMALL:
-            return function(path)
-        return read_once(path, _stamp(status))
-
-    return read
 
 
 class FileWatch:
@@ -69,7 +37,7 @@ class FileWatch:
         return None
 
 
-def _status(path: str | Path) -> os.stat_result | None:
+def _status(path: str) -> os.stat_result | None:
     try:
         return os.stat(path)
     except (OSError, ValueError):  # It may not be a file name.

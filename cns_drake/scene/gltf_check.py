@@ -12,7 +12,6 @@ from typing import Any, NamedTuple
 from urllib.parse import unquote_to_bytes
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from cns_drake.scene.model_finder import resolve
 from evaluation.base import check_expansion, parse_json, read_bytes
@@ -190,6 +189,9 @@ def _own_place(node: Any) -> np.ndarray:
     """Returns the place (4, 4) of a node in its parent."""
     if "matrix" in node:
         return np.array(node["matrix"], dtype=float).reshape(4, 4).T
+    # Slow to import, and most worlds have no such meshes.
+    from scipy.spatial.transform import Rotation
+
     X = np.eye(4)
     X[:3, 3] = node.get("translation", (0, 0, 0))
     X[:3, :3] = Rotation.from_quat(

@@ -7,7 +7,6 @@ and files of all other formats.
 
 import codecs
 from collections import Counter
-from collections.abc import Callable
 from pathlib import Path
 import re
 import struct
@@ -16,7 +15,8 @@ import numpy as np
 
 from cns_drake.scene.collada_check import check_collada
 from cns_drake.scene.gltf_check import check_gltf
-from cns_drake.scene.obj_check import check_obj, unmarked
+from cns_drake.scene.obj_check import unmarked
+from cns_drake.scene.obj_files import ObjFiles
 from cns_drake.scene.ply_check import check_ply
 from evaluation.base import read_bytes
 
@@ -28,7 +28,7 @@ _STL_VERTEX = re.compile(rb"^[ \t]*vertex\b(.*)", re.M | re.I)
 _STL_WORDS = re.compile(rb"^[ \t]*(vertex|endfacet|endsolid)\b", re.M | re.I)
 
 
-def check_mesh_file(path: Path) -> tuple[str, ...]:
+def check_mesh_file(path: Path, objs: ObjFiles) -> tuple[str, ...]:
     """Checks a mesh file; returns notes on what is not read, such as lines.
 
     There is one note for each kind of content that is not read. The tuple is
@@ -40,11 +40,13 @@ def check_mesh_file(path: Path) -> tuple[str, ...]:
         InputError: the file cannot be read.
     """
     ending = path.suffix.lower()
-    if ending in _CHECKS_OF_FILES:
+    if ending == ".obj":
+        return objs.faces(path).notes
+    if ending == ".dae":
         with unmarked(path) as file:
-            return _CHECKS_OF_FILES[ending](file)
+            return check_collada(file)
     if ending not in _CHECKS:
-        formats = " ".join([*_CHECKS, *_CHECKS_OF_FILES])
+        formats = " ".join([*_CHECKS, ".dae", ".obj"])
         raise ValueError(
             f"is no mesh of a format that is read ({formats}); Blender or"
             " trimesh writes these"
@@ -110,11 +112,6 @@ def _is_stl_text(content: bytes) -> bool:
     return content[:5].lower() == b"solid"
 
 
-# File name extension -> function that reads and checks a file.
-_CHECKS_OF_FILES: dict[str, Callable[[Path], tuple[str, ...]]] = {
-    ".dae": check_collada,
-    ".obj": lambda path: check_obj(path).notes,
-}
 # File name extension -> function that checks the contents of a file.
 _CHECKS = {
     **dict.fromkeys(GLTF, check_gltf),

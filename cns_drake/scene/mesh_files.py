@@ -5,20 +5,15 @@ from pathlib import Path
 import tempfile
 
 import numpy as np
-from pydrake.geometry import (
-    Convex,
-    Mesh,
-    MeshSource,
-    ReadObjToTriangleSurfaceMesh,
-)
+from pydrake.geometry import Convex, Mesh, MeshSource
 
 from cns_drake.scene.collada_check import plain_collada
 from cns_drake.scene.drake_errors import PARSER_ERRORS, collected_errors
-from cns_drake.scene.file_watch import once_a_file
 from cns_drake.scene.foreign_meshes import ForeignMeshes
 from cns_drake.scene.gltf_check import plain_gltf
 from cns_drake.scene.mesh_check import GLTF, check_mesh_file, stl_corners
-from cns_drake.scene.obj_check import check_obj, unmarked
+from cns_drake.scene.obj_check import unmarked
+from cns_drake.scene.obj_files import ObjFiles
 from cns_drake.scene.ply_check import has_single_vertices
 from cns_drake.scene.surfaces import LARGEST_SIZE, TriangleSurface
 from evaluation.base import InputError, note, read_bytes, reading
@@ -35,8 +30,9 @@ class MeshFiles:
     All geometries with the same mesh at the same scale share one surface.
     """
 
-    def __init__(self, foreign: ForeignMeshes):
+    def __init__(self, foreign: ForeignMeshes, objs: ObjFiles):
         self._foreign = foreign
+        self._objs = objs
         self._unscaled: dict[object, TriangleSurface] = {}
         self._surfaces: dict[tuple, TriangleSurface] = {}
 
@@ -56,7 +52,7 @@ class MeshFiles:
             # The error alone is enough.
             with reading(Path(place)), collected_errors():
                 surface = (
-                    _read_hull(shape)
+                    _read_hull(shape, self._objs)
                     if isinstance(shape, Convex)
                     else self._read_mesh(shape)
                 )
@@ -94,13 +90,15 @@ class MeshFiles:
         if not path.is_file():
             raise ValueError("no such mesh file")
         ending = path.suffix.lower()
-        check_mesh_file(path)
-        with unmarked(path) as file:
-            p_GVset, triangles, step = (
-                (*_read_obj(file), 0.0)
-                if ending == ".obj"
-                else self._read_foreign(file, path.parent)
-            )
+        check_mesh_file(path, self._objs)
+        step = 0.0
+        if ending == ".obj":
+            p_GVset, triangles = self._objs.surface(path)
+            expected = self._objs.faces(path).num_triangles
+            _check_count(len(triangles), expected)
+        else:
+            with unmarked(path) as file:
+                p_GVset, triangles, step = self._read_foreign(file, path.parent)
         if len(triangles) == 0:
             raise ValueError("holds no triangles")
         # Drake only warns; a ray caster would read outside its memory.
@@ -212,11 +210,11 @@ def _source_key(source: MeshSource) -> object:
     )
 
 
-def _read_hull(shape: Convex) -> TriangleSurface:
+def _read_hull(shape: Convex, objs: ObjFiles) -> TriangleSurface:
     """Returns Drake's convex hull, with the scale applied."""
     source = shape.source()
     if source.is_path():
-        check_mesh_file(Path(source.path()))
+        check_mesh_file(Path(source.path()), objs)
         with unmarked(Path(source.path())) as file:
             # Drake reads the file here.
             hull = Convex(str(file), shape.scale3()).GetConvexHull()
@@ -232,26 +230,3 @@ def _read_hull(shape: Convex) -> TriangleSurface:
     return TriangleSurface(
         np.array(vertices, dtype=float), np.array(triangles, dtype=np.int32)
     )
-
-
-@once_a_file
-def _read_obj(path: Path) -> tuple[np.ndarray, np.ndarray]:
-    """Returns the surface of an OBJ file.
-
-    Returns:
-        Vertices (N, 3), float64 [m], and triangles (M, 3), int32.
-
-    Raises:
-        RuntimeError, ValueError: the file is not a valid OBJ file.
-    """
-    expected = check_obj(path).num_triangles
-    mesh = ReadObjToTriangleSurfaceMesh(path)
-    triangles = np.array(
-        [(t.vertex(0), t.vertex(1), t.vertex(2)) for t in mesh.triangles()],
-        dtype=np.int32,
-    ).reshape(-1, 3)
-    _check_count(len(triangles), expected)
-    p_GVset = np.asarray(mesh.vertices(), dtype=float).reshape(-1, 3)
-    for array in (p_GVset, triangles):
-        array.setflags(write=False)
-    return p_GVset, triangles

@@ -14,7 +14,13 @@ from xml.etree import ElementTree
 from cns_drake.scene.model_finder import ModelFinder, model_file
 from cns_drake.scene.obj_check import check_obj
 from cns_drake.scene.surfaces import LARGEST_SIZE
-from evaluation.base import Element, InputError, read_elements, value_errors
+from evaluation.base import (
+    Element,
+    InputError,
+    read_bytes,
+    read_elements,
+    value_errors,
+)
 
 # File name extensions of models.
 _MODELS = (".sdf", ".world", ".urdf")
@@ -211,7 +217,7 @@ class _ModelCheck:
             self.included.append(file)
         elif file is not None and file.is_file():
             with value_errors(file):
-                check_obj(file)
+                check_obj(read_bytes(file))
 
     def _refuse(self, element: Element, fault: str) -> NoReturn:
         raise InputError(

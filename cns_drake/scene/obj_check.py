@@ -11,7 +11,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cns_drake.scene.file_watch import once_a_file
 from evaluation.base import read_bytes, user_errors
 
 # Statements of OBJ that are read, or that show nothing.
@@ -88,18 +87,16 @@ class ObjFaces(NamedTuple):
     box: np.ndarray | None
 
 
-@once_a_file
-def check_obj(path: Path) -> ObjFaces:
-    """Checks an OBJ file.
+def check_obj(content: bytes) -> ObjFaces:
+    """Checks the content of an OBJ file.
 
     Raises:
         ValueError: a face has a vertex that does not exist, a vertex is not
             made of numbers, or there are surfaces other than faces. The message
             names the line or the statement.
-        InputError: the file cannot be read.
     """
     # Drake accepts carriage returns as line ends, too.
-    content = read_bytes(path).replace(b"\r", b"\n")
+    content = content.replace(b"\r", b"\n")
     if content.startswith(codecs.BOM_UTF8):
         raise ValueError("begins with a byte order mark; save it without")
     counts = _count_ignored(content)

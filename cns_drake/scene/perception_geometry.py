@@ -36,6 +36,7 @@ from pydrake.systems.framework import (
 from cns_drake.scene import surfaces
 from cns_drake.scene.foreign_meshes import ForeignMeshes
 from cns_drake.scene.mesh_files import MeshFiles, mesh_shape_key
+from cns_drake.scene.obj_files import ObjFiles
 from cns_drake.scene.structure_names import part_name, structure_name
 from cns_drake.scene.surfaces import LARGEST_SIZE, Surface, TriangleSurface
 from evaluation.base import InputError, cos, reading, sin
@@ -360,8 +361,12 @@ def read_geometry(
         UserWarning: a deformable geometry is left out, told once.
     """
     found = []
-    with reading(Path("the world's meshes")), ForeignMeshes() as foreign:
-        meshes = MeshFiles(foreign)
+    with (
+        reading(Path("the world's meshes")),
+        ForeignMeshes() as foreign,
+        ObjFiles() as objs,
+    ):
+        meshes = MeshFiles(foreign, objs)
         for record in records:
             if record.is_deformable:
                 _leave_out(record)

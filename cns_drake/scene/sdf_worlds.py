@@ -45,7 +45,7 @@ from cns_drake.scene.model_finder import (
     model_file,
     note_of_missing,
 )
-from cns_drake.scene.obj_check import check_obj
+from cns_drake.scene.obj_files import ObjFiles
 from cns_drake.scene.surfaces import LARGEST_SIZE, MOST_COPIED_TRIANGLES
 from evaluation.base import InputError, check_expansion, value_errors
 
@@ -148,6 +148,7 @@ def read_sdf_world(
     plant: MultibodyPlant,
     path: Path,
     finder: ModelFinder,
+    objs: ObjFiles,
     in_sight: InSight | None = None,
 ) -> tuple[tuple[str, ...], list[UnseenMesh]]:
     """Adds the visuals of a world or model to a plant, all of them static.
@@ -156,6 +157,7 @@ def read_sdf_world(
         plant: plant that is registered with a SceneGraph, and not finalized.
         path: the SDF file.
         finder: finds included models and meshes.
+        objs: reads OBJ files.
         in_sight: tells what is in sight; None if all is.
 
     Returns:
@@ -177,7 +179,7 @@ def read_sdf_world(
     reader = _Reader(path, finder)
     reader.skip("further worlds of the file", len(worlds) - 1)
     reader.add_world(root, world)
-    unseen = [] if in_sight is None else reader.leave_out_unseen(in_sight)
+    unseen = [] if in_sight is None else reader.leave_out_unseen(objs, in_sight)
     reader.register(plant)
     return reader.notes(), unseen
 
@@ -343,32 +345,39 @@ class _Reader:
             self._included[file] = read_model(file, self._finder)
         return self._included[file]
 
-    def leave_out_unseen(self, in_sight: InSight) -> list[UnseenMesh]:
+    def leave_out_unseen(
+        self, objs: ObjFiles, in_sight: InSight
+    ) -> list[UnseenMesh]:
         """Leaves out meshes that are out of sight, and returns them.
 
         The origin of rays is in the middle of the places of all geometry (see
         `ray_casting`), so what is beyond the others' places stays. So do meshes
         whose copies share one surface, and what other poses move.
         """
-        copies = Counter(
-            mesh_shape_key(visual.shape)
+        # Visual -> path and key of its mesh: Drake takes long to tell them.
+        meshes = {
+            id(visual): (
+                str(visual.shape.source().path()),
+                mesh_shape_key(visual.shape),
+            )
             for visuals in self._visuals.values()
             for visual in visuals
             if isinstance(visual.shape, Mesh)
-        )
+        }
+        copies = Counter(key for _, key in meshes.values())
         unseen = []
         for scope, visuals in self._unmoved():
             far: dict[int, UnseenMesh] = {}
             boxes = []
             for visual in visuals:
-                if isinstance(visual.shape, Mesh) and not visual.frame:
-                    path = str(visual.shape.source().path())
-                    number = copies[mesh_shape_key(visual.shape)]
-                    found = _box_of_mesh(path, visual, number)
-                    if found is not None:
-                        name = f"{scope}::{visual.name}"
-                        far[id(visual)] = UnseenMesh(name, path, found[1])
-                        boxes.append(found[0])
+                if id(visual) not in meshes or visual.frame:
+                    continue
+                path, mesh = meshes[id(visual)]
+                found = _box_of_mesh(objs, path, visual, copies[mesh])
+                if found is not None:
+                    name = f"{scope}::{visual.name}"
+                    far[id(visual)] = UnseenMesh(name, path, found[1])
+                    boxes.append(found[0])
             if not far:
                 continue
             for key, is_near in zip(
@@ -797,7 +806,7 @@ class _Reader:
 
 
 def _box_of_mesh(
-    path: str, visual: _Visual, copies: int
+    objs: ObjFiles, path: str, visual: _Visual, copies: int
 ) -> tuple[np.ndarray, tuple[str, ...]] | None:
     """Returns the box (2, 3) of a mesh G in F, and notes about its file.
 
@@ -806,7 +815,7 @@ def _box_of_mesh(
     if not (visual.is_perceived() and path.lower().endswith(".obj")):
         return None
     try:
-        faces = check_obj(Path(path))
+        faces = objs.faces(path)
     except (InputError, ValueError):
         return None  # Whoever reads it tells the fault.
     if faces.box is None or faces.num_triangles == 0:

@@ -104,27 +104,27 @@ def merge_triangles(
         The surface in T; and (M,) int32, for each of the surface's M triangles
         the index that was given with the triangle's geometry.
     """
-    vertices: list[np.ndarray] = [np.zeros((0, 3))]
-    triangles: list[np.ndarray] = [np.zeros((0, 3), np.int32)]
-    owners = [np.zeros(0, np.int32)]
-    num_vertices = 0
-    for index, X_TG, surface in members:
-        R_TG, p = X_TG.rotation().matrix(), surface.p_GVset
+    surfaces = [surface for *_, surface in members]
+    num_vertices = [len(one.p_GVset) for one in surfaces]
+    num_triangles = [len(one.triangles) for one in surfaces]
+    x, y, z = np.concatenate(
+        [np.zeros((0, 3)), *(one.p_GVset for one in surfaces)]
+    ).T
+    X_TGs = np.reshape([X.GetAsMatrix34() for _, X, _ in members], (-1, 3, 4))
+    p_TVset = np.empty((len(x), 3))
+    for axis in range(3):
         # In a fixed order: the result of a matrix library depends on the
         # processor.
-        vertices.append(
-            p[:, :1] * R_TG[:, 0]
-            + p[:, 1:2] * R_TG[:, 1]
-            + p[:, 2:] * R_TG[:, 2]
-            + X_TG.translation()
-        )
-        triangles.append(surface.triangles + np.int32(num_vertices))
-        owners.append(np.full(len(surface.triangles), index, np.int32))
-        num_vertices += len(surface.p_GVset)
-    merged = TriangleSurface(
-        np.concatenate(vertices), np.concatenate(triangles, dtype=np.int32)
+        a, b, c, d = np.repeat(X_TGs[:, axis].T, num_vertices, axis=1)
+        p_TVset[:, axis] = x * a + y * b + z * c + d
+    triangles = np.concatenate(
+        [np.zeros((0, 3), np.int32), *(one.triangles for one in surfaces)],
+        dtype=np.int32,
     )
-    return merged, np.concatenate(owners)
+    first = np.cumsum([0, *num_vertices[:-1]])[: len(surfaces)]
+    triangles += np.repeat(first, num_triangles).astype(np.int32)[:, None]
+    owners = np.array([index for index, *_ in members], np.int32)
+    return TriangleSurface(p_TVset, triangles), np.repeat(owners, num_triangles)
 
 
 def tessellate(surface: Surface, sides: int = _SIDES) -> TriangleSurface:

@@ -23,6 +23,7 @@ from cns_drake.scene.drake_errors import PARSER_ERRORS, collected_errors
 from cns_drake.scene.mesh_check import check_mesh_file
 from cns_drake.scene.model_check import check_model
 from cns_drake.scene.model_finder import ModelFinder
+from cns_drake.scene.obj_files import ObjFiles
 from cns_drake.scene.perception_geometry import anchored_frames, check_shape
 from cns_drake.scene.sdf_worlds import InSight, UnseenMesh, read_sdf_world
 from cns_drake.scene.structure_names import structure_name
@@ -117,8 +118,9 @@ def load_world(
     # plant with many models makes Build() slow.
     plant = MultibodyPlant(time_step=0.0)
     source = plant.RegisterAsSourceForSceneGraph(scene_graph)
+    objs = ObjFiles()
     notes, unseen = _read_world(
-        plant, sdf, [Path(one) for one in model_paths], in_sight
+        plant, sdf, [Path(one) for one in model_paths], objs, in_sight
     )
     _leave_out(scene_graph, source, sdf, without)
     found = _visible_structures(scene_graph)
@@ -130,7 +132,8 @@ def load_world(
             f"LiDAR can see{left_out and f' ({left_out})'}"
         )
     _check_shapes(scene_graph, sdf)
-    notes += _mesh_notes(scene_graph, unseen)
+    with objs:
+        notes += _mesh_notes(scene_graph, unseen, objs)
     vehicle_model = None
     if vehicle is not None:
         vehicle_model = _parse_models(plant, Path(vehicle))[0]
@@ -159,6 +162,7 @@ def _read_world(
     plant: MultibodyPlant,
     path: Path,
     model_paths: Collection[Path],
+    objs: ObjFiles,
     in_sight: InSight | None,
 ) -> tuple[tuple[str, ...], list[UnseenMesh]]:
     """Adds the models of a world to a plant.
@@ -175,7 +179,7 @@ def _read_world(
     with _drake_errors(path):
         if path.suffix.lower() == ".urdf":
             return read_urdf_world(plant, path, finder), []
-        return read_sdf_world(plant, path, finder, in_sight)
+        return read_sdf_world(plant, path, finder, objs, in_sight)
 
 
 def _parse_models(
@@ -306,7 +310,7 @@ def _check_shapes(scene_graph: SceneGraph, sdf: Path) -> None:
 
 
 def _mesh_notes(
-    scene_graph: SceneGraph, unseen: Iterable[UnseenMesh]
+    scene_graph: SceneGraph, unseen: Iterable[UnseenMesh], objs: ObjFiles
 ) -> tuple[str, ...]:
     """Returns notes about content of the meshes that is not read.
 
@@ -326,7 +330,7 @@ def _mesh_notes(
         with value_errors(path):
             found = known.get(path)
             if found is None:
-                found = check_mesh_file(Path(path))
+                found = check_mesh_file(Path(path), objs)
             notes += [f"{path}: {one}" for one in found]
     return tuple(notes)
 

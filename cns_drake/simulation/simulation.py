@@ -1,20 +1,17 @@
 """Running a scenario from its first to its last frame."""
 
+from __future__ import annotations
+
 from collections.abc import Callable
 from dataclasses import dataclass
 import math
 from pathlib import Path
 import time
+from typing import TYPE_CHECKING
 
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import Context, Diagram
 
-from cns_drake.pictures import (
-    MeshcatRecorder,
-    ShownStages,
-    other_stage,
-    read_drive_page,
-)
 from cns_drake.recording import (
     START_NS,
     BackgroundWriter,
@@ -56,6 +53,9 @@ from evaluation.base import (
     interrupts_wait,
     write_text,
 )
+
+if TYPE_CHECKING:
+    from cns_drake.pictures import MeshcatRecorder
 
 # Reports how many frames of how many are done.
 ProgressCallback = Callable[[int, int], None]
@@ -148,6 +148,8 @@ def simulate(
         if beside is not None:
             if page_file is None:
                 raise InputError("beside: only with a page")
+            from cns_drake.pictures import read_drive_page
+
             other = read_drive_page(Path(beside), _city(scenario))
         RecordingFolder(folder).check(overwrite)
         check_folder_writable(folder.parent)
@@ -280,6 +282,9 @@ def _fingerprint(drive: LoadedDrive, inputs: dict[str, str]) -> str:
 
 
 def _make_page(drive: LoadedDrive, in_sight: InSight | None) -> MeshcatRecorder:
+    # Slow to import, and most drives have no page.
+    from cns_drake.pictures import MeshcatRecorder, ShownStages, other_stage
+
     scenario = drive.scenario
     other, other_name, is_earlier = other_stage(scenario)
     stage = scenario.stage

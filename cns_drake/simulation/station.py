@@ -1,6 +1,9 @@
 """The Diagram of a scenario: the only place where systems are connected."""
 
+from __future__ import annotations
+
 from collections.abc import Mapping
+from typing import TYPE_CHECKING
 
 import numpy as np
 from pydrake.common.value import AbstractValue, Value
@@ -18,7 +21,6 @@ from pydrake.systems.framework import (
 from pydrake.systems.rendering import MultibodyPositionToGeometryPose
 
 from cns_drake.motion import VehicleMotion, VehicleSweep
-from cns_drake.pictures import MeshcatRecorder
 from cns_drake.ray_casting import KnownPoses
 from cns_drake.recording import (
     START_NS,
@@ -41,6 +43,9 @@ from cns_drake.sensors import (
 from cns_drake.simulation.loaded_drive import LoadedDrive, load_drive
 from cns_drake.simulation.sensor_recording import connect_by_name
 from cns_drake.traffic import TrafficMotion, add_traffic, connect_traffic
+
+if TYPE_CHECKING:
+    from cns_drake.pictures import MeshcatRecorder
 
 
 def make_station(

@@ -8,6 +8,7 @@ contains the definitions of its message types.
 
 from collections.abc import Mapping
 import dataclasses
+import functools
 from pathlib import Path
 from typing import Any
 
@@ -33,23 +34,22 @@ COMPRESSED_IMAGE = "sensor_msgs/msg/CompressedImage"
 DETECTIONS_3D = "vision_msgs/msg/Detection3DArray"
 SCENE_UPDATE = "foxglove_msgs/msg/SceneUpdate"
 
-_TYPESTORE = get_typestore(Stores.ROS2_HUMBLE)
 _FOLDER = Path(__file__).with_name("messages")
-for _path in sorted(_FOLDER.glob("*/msg/*.msg")):
-    _name = _path.relative_to(_FOLDER).with_suffix("").as_posix()
-    _TYPESTORE.register(
-        get_types_from_msg(_path.read_text(encoding="utf-8"), _name)
-    )
 
 
+@functools.cache
 def known_types() -> Typestore:
-    """Returns the table of message types."""
-    return _TYPESTORE
+    """Returns the table of message types, which takes long to make."""
+    types = get_typestore(Stores.ROS2_HUMBLE)
+    for path in sorted(_FOLDER.glob("*/msg/*.msg")):
+        name = path.relative_to(_FOLDER).with_suffix("").as_posix()
+        types.register(get_types_from_msg(path.read_text("utf-8"), name))
+    return types
 
 
 def message_class(message_type: str) -> type:
     """Returns the Python class of a message type."""
-    return _TYPESTORE.types[message_type]
+    return known_types().types[message_type]
 
 
 def make_message(message_type: str, **fields: Any) -> Any:
@@ -59,7 +59,7 @@ def make_message(message_type: str, **fields: Any) -> Any:
     itself a message can be a message, a mapping of that message's fields, or a
     sequence of all its fields.
     """
-    _, kinds = _TYPESTORE.fielddefs[message_type]
+    _, kinds = known_types().fielddefs[message_type]
     values = {
         name: _field_value(kind, fields.pop(name, None)) for name, kind in kinds
     }
@@ -73,7 +73,7 @@ def _field_value(kind: tuple, given: Any) -> Any:
         if dataclasses.is_dataclass(given):
             return given
         if given is not None and not isinstance(given, Mapping):
-            names = [name for name, _ in _TYPESTORE.fielddefs[inner][1]]
+            names = [name for name, _ in known_types().fielddefs[inner][1]]
             given = dict(zip(names, given, strict=True))
         return make_message(inner, **(given or {}))
     if node is Nodetype.BASE:
@@ -92,18 +92,20 @@ def _field_value(kind: tuple, given: Any) -> Any:
 
 def message_definition(message_type: str) -> str:
     """Returns the .msg text of a type and of all types that it contains."""
-    text, _ = _TYPESTORE.generate_msgdef(message_type, ros_version=2)
+    text, _ = known_types().generate_msgdef(message_type, ros_version=2)
     return text
 
 
 def message_hash(message_type: str) -> str:
     """Returns the hash of a message type in REP-2011 form (`RIHS01_...`)."""
-    return _TYPESTORE.hash_rihs01(message_type)
+    return known_types().hash_rihs01(message_type)
 
 
 def serialize(message: Any) -> bytes:
     """Returns a message, also one of ROS 1, serialised as CDR."""
-    return bytes(_TYPESTORE.serialize_cdr(message, _known(message.__msgtype__)))
+    return bytes(
+        known_types().serialize_cdr(message, _known(message.__msgtype__))
+    )
 
 
 def deserialize(data: bytes | memoryview, message_type: str) -> Any:
@@ -112,7 +114,7 @@ def deserialize(data: bytes | memoryview, message_type: str) -> Any:
     Raises:
         Exception: of any class, if the data are not a message of this type.
     """
-    return _TYPESTORE.deserialize_cdr(data, _known(message_type))
+    return known_types().deserialize_cdr(data, _known(message_type))
 
 
 def _known(message_type: str) -> str:

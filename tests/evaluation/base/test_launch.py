@@ -38,3 +38,27 @@ def test_an_interrupt_in_a_destructor_ends_the_program(number, when):
     assert ended.returncode == 130
     assert ended.stdout == "loading\n"
     assert ended.stderr == "program: interrupted\n"
+
+
+LAST = """
+import atexit, gc
+from evaluation.base import start
+
+def run():
+    gc.callbacks.append(lambda phase, facts: print(phase, facts))
+    atexit.register(lambda: print("the end"))
+    cycle = []
+    cycle.append(cycle)
+
+start("program", lambda: run)
+"""
+
+
+@pytest.mark.slow
+def test_no_garbage_is_looked_for_at_the_end():
+    ended = subprocess.run(
+        [sys.executable, "-c", LAST], capture_output=True, text=True, check=True
+    )
+    # Python still looks, where nothing is left: the cycle stays.
+    assert ended.stdout.startswith("the end\nstart ")
+    assert "stop {'generation': 2, 'collected': 0," in ended.stdout

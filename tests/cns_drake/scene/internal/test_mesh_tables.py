@@ -20,6 +20,7 @@ import pytest
 
 from cns_drake.scene.foreign_meshes import ForeignMeshes
 from cns_drake.scene.mesh_files import MeshFiles
+from cns_drake.scene.obj_files import ObjFiles
 from evaluation.base import InputError
 
 PAGE = Path(__file__).parents[4] / "docs" / "formats.md"
@@ -28,7 +29,7 @@ PAGE = Path(__file__).parents[4] / "docs" / "formats.md"
 @pytest.fixture(scope="module")
 def files():
     with ForeignMeshes() as foreign:
-        yield MeshFiles(foreign)
+        yield MeshFiles(foreign, ObjFiles())
 
 
 def obj_with(tag):
