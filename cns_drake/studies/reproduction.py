@@ -35,7 +35,12 @@ from evaluation.base import (
 from evaluation.drives import driven_way
 from evaluation.recognition import RetrievalProtocol, choose_methods
 from evaluation.results import PrintStyle
-from evaluation.study import RecordingInfo, scenario_digest, study_recordings
+from evaluation.study import (
+    RecordingInfo,
+    check_study_output,
+    scenario_digest,
+    study_recordings,
+)
 from worlds.maps import MapFolder, recordable_map, recordable_maps
 
 # Mean size of a page.
@@ -103,6 +108,7 @@ def reproduce_maps(
             pictures += _plan_pictures(folder, output / "pictures")
     pages = {s.name: output / "pages" / f"{s.name}.html" for s in drives}
     every = [*drives, *controls]
+    check_study_output(output / "report")
     make_folder(output)
     space: Space | None = _expected_space(
         usual_frames(every),

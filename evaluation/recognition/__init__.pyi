@@ -16,7 +16,7 @@ from .drive_data import DriveData as DriveData
 from .drive_data import Map as Map
 from .drive_data import Picture as Picture
 from .drive_data import asked_key as asked_key
-from .drive_data import read_drive as read_drive
+from .drive_data import gathered as gathered
 from .metrics import METRICS as METRICS
 from .metrics import Metric as Metric
 from .metrics import Mode as Mode

@@ -263,7 +263,7 @@ class DriveData:
         if (store := self.store) is None or not (missing := self.missing()):
             return
         make_folder(store.folder)
-        found = read_drive(self.source(), missing, store.folder)
+        found = gathered(self.source(), missing, store.folder)
         doing("writing maps and descriptors")
         for one, value in found.items():
             store.write(self.key(one), value)
@@ -280,7 +280,7 @@ class DriveData:
             part = self.store.part(self.key(one))
             return part.read, part.size()
         if self._found is None:
-            self._found = read_drive(self.source(), self.asked)
+            self._found = gathered(self.source(), self.asked)
         value = self._found.pop(one)
         of_places = getattr(getattr(value, "places", None), "descriptors", None)
         return lambda: value, getattr(of_places, "num_bytes", 0)
@@ -296,7 +296,7 @@ def asked_key(drive: str, one: Asked) -> Key:
     return Key(kind, {"drive": drive, **one.identity()}, _VERSION)
 
 
-def read_drive(
+def gathered(
     recording: Drive, asked: Collection[Asked], folder: Path | None = None
 ) -> dict[Asked, Any]:
     """Returns all that is asked of a drive; each scan is read once, in order.

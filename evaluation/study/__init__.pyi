@@ -32,6 +32,7 @@ from .recordings.map_drives import scenario_digest as scenario_digest
 from .recordings.recorded_pairs import recorded_pairs as recorded_pairs
 from .recordings.recording_search import find_recordings as find_recordings
 from .study import Study as Study
+from .study import check_study_output as check_study_output
 from .tasks.change import ChangeTask as ChangeTask
 from .tasks.localise import LocaliseTask as LocaliseTask
 from .tasks.map import MapTask as MapTask

@@ -117,10 +117,7 @@ class Study(ExperimentRun):
             for name, settings in wanted.items()
         }
         self._check_charts()
-        check_output(self.output, ["page"])
-        for folder in (self.store.folder, self.figures):
-            if os.path.lexists(folder) and not folder.is_dir():
-                raise InputError(f"{folder}: not a folder")
+        check_study_output(self.output)
         self._note_lower_levels()
 
     @property
@@ -382,6 +379,22 @@ def _worlds(pairs: Iterable[Pair]) -> list[str]:
         if one.world is not None
     )
     return list(dict.fromkeys(found))
+
+
+def check_study_output(output: Path) -> None:
+    """Checks before all work what stands in the way of a study's files.
+
+    Args:
+        output: folder of the study.
+
+    Raises:
+        InputError: `check_output` refuses the folder, or a file has the name of
+            one of its folders.
+    """
+    check_output(output, ["page"])
+    for folder in (output / "parts", output / "figures"):
+        if os.path.lexists(folder) and not folder.is_dir():
+            raise InputError(f"{folder}: not a folder")
 
 
 def _condition(one: Pair, factors: Mapping[str, Any]) -> tuple[object, ...]:

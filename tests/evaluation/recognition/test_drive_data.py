@@ -16,7 +16,7 @@ from evaluation.recognition import (
     asked_of_places,
     asked_of_queries,
     choose_methods,
-    read_drive,
+    gathered,
 )
 
 pytestmark = pytest.mark.slow
@@ -72,14 +72,14 @@ def found(folder):
         return scan(index)
 
     recorded.scan = once
-    found = read_drive(recorded, ASKED)
+    found = gathered(recorded, ASKED)
     assert len(read) == len(recorded)
     return found
 
 
 def test_each_is_what_is_found_alone(folder, found):
     for one in ASKED:
-        assert_equal(read_drive(open_drive(folder), [one])[one], found[one])
+        assert_equal(gathered(open_drive(folder), [one])[one], found[one])
 
 
 def test_maps_are_those_of_which_the_tcr_is_measured(folder, found):

@@ -1314,10 +1314,7 @@ def offered_readers():
     found |= {f"data set {name}" for name in data_sets()}
     found |= {f"source {one.title}" for one in map_sources()}
     found |= {f"cloud {ending}" for ending in cloud_files._READERS}
-    meshes = {
-        *mesh_check._CHECKS,
-        *mesh_check._CHECKS_OF_FILES,
-    }
+    meshes = {*mesh_check._CHECKS, ".dae", ".obj"}
     found |= {f"mesh {ending}" for ending in meshes}
     return found | {"world .sdf", "world .urdf"}
 
