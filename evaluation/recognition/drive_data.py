@@ -226,7 +226,8 @@ def kept_points(scan: np.ndarray, half_extent: float) -> np.ndarray:
 class DriveData:
     """A drive that is read once for all that is asked of it.
 
-    What was read is in memory until it is taken; with a store, it is in files.
+    What was read is in memory, descriptors until they are taken; with a store,
+    it is in files.
 
     Attributes:
         source: opens the drive.
@@ -271,7 +272,7 @@ class DriveData:
     def reader(self, one: Asked) -> tuple[Callable[[], Any], float]:
         """Returns a function that returns something asked, and its size.
 
-        What is in memory leaves it with this function.
+        Descriptors that are in memory leave it with this function.
 
         Returns:
             The function; approximate size of its result [bytes].
@@ -281,12 +282,15 @@ class DriveData:
             return part.read, part.size()
         if self._found is None:
             self._found = gathered(self.source(), self.asked)
-        value = self._found.pop(one)
+        # Others than descriptors are small, or are asked for more than once.
+        value = self._found[one]
+        if isinstance(one, Descriptors):
+            del self._found[one]
         of_places = getattr(getattr(value, "places", None), "descriptors", None)
         return lambda: value, getattr(of_places, "num_bytes", 0)
 
     def take(self, one: Asked) -> Any:
-        """Returns something asked; it leaves the memory."""
+        """Returns something asked; descriptors leave the memory."""
         return self.reader(one)[0]()
 
 

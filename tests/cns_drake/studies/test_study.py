@@ -334,6 +334,17 @@ def test_a_setting_is_compared_with_that_of_the_baseline(
         assert (control.value, math.isnan(control.low)) == (1.0, True)
 
 
+def test_a_drive_is_compared_with_itself(town, tmp_path, jobs_done):
+    """The only pair: its one drive is read into memory."""
+    wanted = experiment(
+        town,
+        tasks={"change": {"spacing": 5}, "place": {}},
+        protocol={"base": "recorded", "query_spacing": 5, "place_spacing": 5},
+    )
+    found = values(measure(wanted, tmp_path), task="change")
+    assert found["tcr_sym"] == 0.0
+
+
 def test_an_unchanged_city_has_no_change(town, tmp_path, jobs_done):
     wanted = experiment(
         town,
