@@ -459,3 +459,19 @@ def test_a_sector_that_is_none_is_refused(hidden):
         load_scenario("suburbia_01").with_fields(
             {"lidars": {"*": {"hidden_deg": hidden}}}, "mine"
         )
+
+
+def test_a_drive_goes_through_the_city_of_another(small_map, tmp_path):
+    """Also if the city was made for one of them."""
+    drive = make_scenario(scenario_values(small_map), "test")
+    aged = drive.in_folder((tmp_path / "aged", "02"))
+    back = aged.in_city_of(drive)
+    assert (back.folder.path, back.stage_in_folder) == (
+        drive.folder.path,
+        drive.stage_in_folder,
+    )
+    there = drive.in_city_of(aged)
+    assert (there.folder.path, there.stage_in_folder) == (
+        tmp_path / "aged",
+        "02",
+    )
