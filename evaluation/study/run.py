@@ -54,13 +54,20 @@ def measure_pairs(
             error names all of them.
     """
     left = [one for one in _alike(pairs, store) if not one.is_done()]
-    drives = _drives_of(left, shown, store)
+    asked = {one: tuple(one.asks()) for one in left}
+    drives = _drives_of(asked, shown, store)
     readings = _jobs(
         (one.words, ReadDrive(one, data))
         for one, data in drives.values()
         if data.store is not None
     )
-    steps = [one.reading(drives) for one in left]
+    steps = [
+        replace(
+            one,
+            drives={drive.digest: drives[drive.digest][1] for drive, _ in some},
+        )
+        for one, some in asked.items()
+    ]
     told = forecast([*readings, *_measurements(steps)], cluster, space)
     if told is not None:
         on_note(f"{told}; after an interruption, run the same command again")
@@ -131,35 +138,27 @@ class MeasurePair(Step):
     @property
     def output(self) -> Path:
         # Tasks lock the files of results that several pairs share.
-        return self.store.folder / "pairs" / next(self._keys()).digest
+        return (
+            self.store.folder / "pairs" / next(self._keys(self.tasks[0])).digest
+        )
 
     def is_done(self) -> bool:
-        return all(map(self.store.has, self._keys()))
+        return not any(self._left())
 
     def run(self, reporter: Reporter) -> None:
-        for task in self.tasks:
-            keys = (key for pair in self.pairs for key in task.keys(pair))
-            if not all(map(self.store.has, keys)):
-                task.measure(
-                    self.pairs,
-                    lambda drive: self.drives[drive.digest],
-                    self.store,
-                    reporter,
-                )
+        for task in self._left():
+            task.measure(
+                self.pairs,
+                lambda drive: self.drives[drive.digest],
+                self.store,
+                reporter,
+            )
 
     def asks(self) -> Iterator[DriveAsked]:
         """Yields what the tasks that are left ask of drives."""
-        for task in self.tasks:
+        for task in self._left():
             for pair in self.pairs:
                 yield from task.asks(pair, self.store)
-
-    def reading(
-        self, drives: Mapping[str, tuple[StudyDrive, DriveData]]
-    ) -> "MeasurePair":
-        """Returns the step with what has been asked of its drives."""
-        own = dict.fromkeys(drive.digest for drive, _ in self.asks())
-        found = {digest: drives[digest][1] for digest in own}
-        return replace(self, drives=found)
 
     def lacks_drives(self) -> bool:
         """Returns whether a drive was to be read for it, and was not."""
@@ -168,10 +167,15 @@ class MeasurePair(Step):
             for one in self.drives.values()
         )
 
-    def _keys(self) -> Iterator[Key]:
+    def _left(self) -> Iterator[Task]:
+        """Yields the tasks of which a result is not in the store."""
         for task in self.tasks:
-            for pair in self.pairs:
-                yield from task.keys(pair)
+            if not all(map(self.store.has, self._keys(task))):
+                yield task
+
+    def _keys(self, task: Task) -> Iterator[Key]:
+        for pair in self.pairs:
+            yield from task.keys(pair)
 
 
 def _alike(
@@ -196,11 +200,17 @@ def _alike(
 
 
 def _drives_of(
-    groups: Iterable[MeasurePair], shown: Iterable[DriveAsked], store: Store
+    groups: Mapping[MeasurePair, Iterable[DriveAsked]],
+    shown: Iterable[DriveAsked],
+    store: Store,
 ) -> dict[str, tuple[StudyDrive, DriveData]]:
     """Returns the drives to read, by digest, with what is asked of them.
 
     What several pairs need, or what may not fit into memory, is in the store.
+
+    Args:
+        groups: the pairs, with what each asks of drives.
+        shown: see `measure_pairs`.
     """
     asked: dict[str, tuple[StudyDrive, dict[Asked, None]]] = {}
     stored: set[str] = set()
@@ -208,9 +218,9 @@ def _drives_of(
     def ask(drive: StudyDrive, one: Asked) -> None:
         asked.setdefault(drive.digest, (drive, {}))[1][one] = None
 
-    for group in groups:
+    for group, some in groups.items():
         before = {*asked}
-        for drive, one in group.asks():
+        for drive, one in some:
             if drive.digest in before:
                 stored.add(drive.digest)
             ask(drive, one)
@@ -222,8 +232,8 @@ def _drives_of(
         stored.add(drive.digest)
         ask(drive, one)
     found = {}
-    for digest, (drive, some) in asked.items():
-        data = DriveData(drive.source, tuple(some), digest, store)
+    for digest, (drive, every) in asked.items():
+        data = DriveData(drive.source, tuple(every), digest, store)
         if digest not in stored and data.missing():
             data = replace(data, store=None)
         found[digest] = drive, data

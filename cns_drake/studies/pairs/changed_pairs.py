@@ -5,16 +5,13 @@ from collections.abc import Callable, Sequence
 from cns_drake.scenarios import Scenario, city_step, make_maps
 from cns_drake.studies.drives.named_stages import MissingError
 from cns_drake.studies.maps.experiment_maps import MapPairs
-from cns_drake.studies.pairs.comparisons import PairMaker
+from cns_drake.studies.pairs.comparisons import QUERY_SCANS, PairMaker
 from cns_drake.studies.pairs.map_upkeep import UpkeptSource, plain_source
 from evaluation.base import fingerprint
 from evaluation.map_update import NOT_MAINTAINED
 from evaluation.recognition import KEEP_ALL
 from evaluation.results import CAUSE
 from evaluation.study import ExperimentRun, Pair
-
-# Fields of the protocol that change the scans of queries.
-_QUERY_SCANS = ("turn_queries", "tilt_queries", "hide_sector")
 
 
 def changed_pairs(
@@ -74,7 +71,7 @@ def pair_fingerprint(pair: Pair, drives: Sequence[Scenario]) -> str:
     is_one = not beside and pair.keep == KEEP_ALL
     of_cause = {
         name: getattr(pair.protocol, name)
-        for name in _QUERY_SCANS
+        for name in QUERY_SCANS
         if getattr(pair.protocol, name) != getattr(pair.stated, name)
     }
     if of_cause:

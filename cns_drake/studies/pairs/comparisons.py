@@ -44,7 +44,7 @@ from evaluation.study import (
 )
 
 # Fields of the protocol that change the scans of the queries at random.
-_QUERY_SCANS = ("turn_queries", "tilt_queries", "hide_sector")
+QUERY_SCANS = ("turn_queries", "tilt_queries", "hide_sector")
 # Greatest length of a value in the name of a drive, which names its folder.
 _LONGEST_LABEL = 48
 
@@ -356,7 +356,7 @@ class PairMaker:
         protocol = fields.get("protocol", {})
         found = {
             name: protocol[name]
-            for name in _QUERY_SCANS
+            for name in QUERY_SCANS
             if name in protocol and name not in stated
         }
         return {**found, "seed": seed} if found else {}

@@ -1,12 +1,12 @@
 """The task `map`: scores of change detectors on the maps of two drives."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from importlib.util import find_spec
 from pathlib import Path
 import tempfile
 
 from cns_drake.ground_truth import labelled_drive, write_truth
-from evaluation.base import Key, Reporter, Store
+from evaluation.base import Key, Reporter
 from evaluation.drives import DriveSource
 from evaluation.map_update import BASELINES, TRUTH, MapScores, score_methods
 from evaluation.study import DataOf, MapTask, Pair
@@ -27,23 +27,16 @@ class DrivenMapTask(MapTask):
         }
         return [Key(self.name, made_of, self.version)]
 
-    def measure(
-        self,
-        pairs: Sequence[Pair],
-        data_of: DataOf,
-        store: Store,
-        reporter: Reporter,
-    ) -> None:
-        pair = pairs[0]
-        found = measure_maps(
+    def compute(
+        self, pair: Pair, data_of: DataOf, reporter: Reporter
+    ) -> dict[str, MapScores]:
+        return measure_maps(
             reporter,
             pair.database[0].source,
             pair.query.source,
             self._names,
             float(self.settings["spacing"]),
         )
-        (key,) = self.keys(pair)
-        store.write(key, found)
 
     @property
     def _names(self) -> tuple[str, ...]:

@@ -204,9 +204,7 @@ class SeenTask(Task):
         reporter: Reporter,
     ) -> None:
         pair = pairs[0]
-        if not (keys := self.keys(pair)):
-            return
-        *sightings, events = keys
+        *sightings, events = self.keys(pair)
         first, *_ = sources = [
             plain_source(one.source) for one in (*pair.database, pair.query)
         ]

@@ -1,10 +1,10 @@
 """The task `change`: how much the city changed between two drives."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from typing import Any, ClassVar
 
 from evaluation.base import Key, Reporter, Store
-from evaluation.change import DriveMap, change_of_maps
+from evaluation.change import ChangeReport, DriveMap, change_of_maps
 from evaluation.recognition import Asked, Map
 from evaluation.study.pair import Pair, StudyDrive
 from evaluation.study.tasks.task import DataOf, Task, check_positive
@@ -28,9 +28,8 @@ class ChangeTask(Task):
     def asks(
         self, pair: Pair, store: Store
     ) -> Iterator[tuple[StudyDrive, Asked]]:
-        if not all(map(store.has, self.keys(pair))):
-            for drive in self._drives(pair):
-                yield drive, Map(self.settings["spacing"])
+        for drive in self._drives(pair):
+            yield drive, Map(self.settings["spacing"])
 
     def keys(self, pair: Pair) -> list[Key]:
         drives = self._drives(pair)
@@ -40,26 +39,19 @@ class ChangeTask(Task):
         }
         return [Key(self.name, made_of, self.version)] if drives else []
 
-    def measure(
-        self,
-        pairs: Sequence[Pair],
-        data_of: DataOf,
-        store: Store,
-        reporter: Reporter,
-    ) -> None:
-        maps = [
-            data_of(drive).take(asked)
-            for drive, asked in self.asks(pairs[0], store)
-        ]
-        if maps:
-            # Without the spread over shifted grids, which would take sixteen
-            # times as long as all other computations.
-            first, last = (
-                DriveMap(one.name, one.voxels, one.X_WS[:, :3, 3])
-                for one in maps
-            )
-            (key,) = self.keys(pairs[0])
-            store.write(key, change_of_maps(first, last))
+    def compute(
+        self, pair: Pair, data_of: DataOf, reporter: Reporter
+    ) -> ChangeReport:
+        # Without the spread over shifted grids, which would take sixteen times
+        # as long as all other computations.
+        maps = (
+            data_of(drive).take(Map(self.settings["spacing"]))
+            for drive in self._drives(pair)
+        )
+        first, last = (
+            DriveMap(one.name, one.voxels, one.X_WS[:, :3, 3]) for one in maps
+        )
+        return change_of_maps(first, last)
 
     def _drives(self, pair: Pair) -> tuple[StudyDrive, ...]:
         """Returns the two drives that are compared; none to measure nothing."""

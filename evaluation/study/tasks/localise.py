@@ -6,7 +6,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from evaluation.base import InputError, Key, Reporter, Store, file_digests
+from evaluation.base import InputError, Key, Reporter, file_digests
 from evaluation.drives import JoinedSource
 from evaluation.localisation import (
     KISS_MATCHER,
@@ -88,19 +88,14 @@ class LocaliseTask(Task):
         }
         return [Key(self.name, made_of, self.version)]
 
-    def measure(
-        self,
-        pairs: Sequence[Pair],
-        data_of: DataOf,
-        store: Store,
-        reporter: Reporter,
-    ) -> None:
-        pair = pairs[0]
+    def compute(
+        self, pair: Pair, data_of: DataOf, reporter: Reporter
+    ) -> list[np.ndarray]:
         database = pair.database[0].source
         if pair.is_composed:
             sources = tuple(one.source for one in pair.database)
             database = JoinedSource(sources, pair.keep)
-        found = measure_localisation(
+        return measure_localisation(
             reporter,
             database,
             pair.query.source,
@@ -113,8 +108,6 @@ class LocaliseTask(Task):
             tuple(self.settings["estimator"].items()),
             self.settings["odometry_drift"],
         )
-        (key,) = self.keys(pair)
-        store.write(key, found)
 
     def _named_results(
         self, found: Sequence[np.ndarray]

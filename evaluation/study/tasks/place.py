@@ -52,8 +52,6 @@ class _RecognitionTask(Task):
         reporter: Reporter,
     ) -> None:
         left = self._left(pairs, store)
-        if not left:
-            return
         pair = pairs[0]
         compared = PlaceComparison(
             tuple(map(data_of, pair.database)),

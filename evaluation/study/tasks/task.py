@@ -118,7 +118,6 @@ class Task(abc.ABC):
         There are none if the task does not apply to the pair.
         """
 
-    @abc.abstractmethod
     def measure(
         self,
         pairs: Sequence[Pair],
@@ -127,6 +126,9 @@ class Task(abc.ABC):
         reporter: Reporter,
     ) -> None:
         """Adds the results that are missing to the store.
+
+        It is called only if some are missing. By default a task has one result,
+        which `compute` returns.
 
         Args:
             pairs: pairs that differ only in the radius of a match.
@@ -137,6 +139,14 @@ class Task(abc.ABC):
         Raises:
             InputError: a drive cannot be read, or a method fails.
         """
+        (key,) = self.keys(pairs[0])
+        store.write(key, self.compute(pairs[0], data_of, reporter))
+
+    def compute(
+        self, pair: Pair, data_of: DataOf, reporter: Reporter
+    ) -> object:
+        """Returns the only result; a task with several defines `measure`."""
+        raise NotImplementedError
 
     def found(self, pair: Pair, store: Store) -> Any:
         """Returns the task's result for a pair of drives, once it is measured.
